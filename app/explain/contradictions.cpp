@@ -68,7 +68,7 @@ std::vector<LostMarker> lost_of_free_markers(const Explanation& now, const Evide
       return std::ranges::find(free, id) != free.end() && (at_s < middle_s) != first;
     });
     std::vector<std::string> said;
-    const Explanation other = explained(half.view(), options, said);
+    const Explanation other = explained_part(half.view(), options, said);
     if (!is_settled(other) || !other.structure ||
         other.structure->free_markers.size() >= free.size())
       continue;

@@ -48,18 +48,6 @@ std::string words_of(const std::vector<ReadingApart>& readings, const Explanatio
   return shown ? fmt::format("{}; the markers say {:.6g}", out, *shown) : out;
 }
 
-// A part of the evidence may lack what was declared: then it is no rival of the whole.
-Explanation explained_part(const ChangedEvidence& part, const ExplainOptions& options,
-                           std::vector<std::string>& said) {
-  try {
-    return explained(part.view(), options, said);
-  } catch (const Error& error) {
-    Explanation out;
-    out.failure = error;
-    return out;
-  }
-}
-
 // Without the readings that nothing leads to, unless the markers speak for them.
 Explanation with_odd_readings_apart(const Evidence& evidence,
                                     const std::vector<ReadingApart>& apart,
@@ -69,7 +57,7 @@ Explanation with_odd_readings_apart(const Evidence& evidence,
   const ChangedEvidence changed = without(evidence, apart);
   std::vector<std::string> said;
   std::vector<std::string> said_with_them;
-  Explanation without_them = explained_part(changed, options, said);
+  Explanation without_them = explained_part(changed.view(), options, said);
   // What needed no sighting to be given up has nothing against it.
   const bool cost_nothing =
       sightings_in(changed.observed.measurements) == sightings_in(evidence.observed.measurements);
@@ -152,7 +140,7 @@ Explanation with_contradictions_apart(Explanation now, const Evidence& evidence,
     kept[i] = std::move(found->words_if_kept);
     if (!found->without_it) continue;
     std::vector<std::string> said;
-    Explanation other = explained_part(*found->without_it, alike, said);
+    Explanation other = explained_part(found->without_it->view(), alike, said);
     const bool is_enough = found->is_no_error_of_robot && is_settled(other);
     if (!is_enough && !is_better(other, now, evidence.observed.measurements)) continue;
     now = std::move(other);

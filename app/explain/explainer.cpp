@@ -404,4 +404,15 @@ Explanation explained(const Evidence& evidence, const ExplainOptions& options,
   return Explainer(evidence, options).explained(warnings);
 }
 
+Explanation explained_part(const Evidence& part, const ExplainOptions& options,
+                           std::vector<std::string>& warnings) {
+  try {
+    return explained(part, options, warnings);
+  } catch (const Error& error) {
+    Explanation out;
+    out.failure = error;
+    return out;
+  }
+}
+
 }  // namespace kinescope

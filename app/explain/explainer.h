@@ -14,4 +14,8 @@ namespace kinescope {
 [[nodiscard]] Explanation explained(const Evidence& evidence, const ExplainOptions& options,
                                     std::vector<std::string>& warnings);
 
+/// The same of a part of it, which may lack what was declared: then only why.
+[[nodiscard]] Explanation explained_part(const Evidence& part, const ExplainOptions& options,
+                                         std::vector<std::string>& warnings);
+
 }  // namespace kinescope
